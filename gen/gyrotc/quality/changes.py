@@ -1,24 +1,22 @@
 """Changes of a rate that neither temperature, its rate, nor noise explains: one search in one likelihood (`fits`).
 
-Every place of every run is tried for a step, a transition of a duration, a rate that is displaced and comes back, and a
-drift that begins. What may be clear is fitted, all changes found are placed anew beside one another, those that cannot
-be clear any more are dropped, and the search goes on in what is left. Then the noise is estimated anew beside what was
-found, since a change hides in a noise that is estimated with it, and all is done once more: now a change must be clear.
-The level is controlled over all places of all runs together (Bonferroni): chance makes a change in one of two hundred
-sets. See Basseville and Nikiforov, Detection of Abrupt Changes, 1993, 2.2 and 4.
+Every place of every run is tried for a step, a transition of a duration, a departure that comes back, and a drift that
+begins. What is clear is fitted, all changes found are placed anew beside one another, those that are not clear any more
+are dropped, and the search goes on in what is left; then the noise is estimated anew beside what was found, and all is
+done once more. The level is controlled over all places of all runs together (Bonferroni): chance makes a change in one
+of two hundred sets. See Basseville and Nikiforov, Detection of Abrupt Changes, 1993, 2.2 and 4.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
 
-from ..common.arrays import BoolArray, FloatArray, parts_of
+from ..common.arrays import FloatArray, parts_of
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, noise_of
 from .findings import ValueWithLimits
 from .fits import (
@@ -38,7 +36,7 @@ from .fits import (
     run_cells,
 )
 
-RateChangeKind = Literal["step", "transition", "drift", "gain", "displaced"]
+RateChangeKind = Literal["step", "transition", "drift", "gain"]
 _Tried = tuple[str, float]
 """Shape that the search tries: kind, and how long it lasts, s."""
 
@@ -51,10 +49,8 @@ _STEP_S = 30.0  # what takes no longer is a step
 # From a step to ten minutes, where a drift begins
 _DURATIONS_S = (0.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0)
 _TRIED_S = (0.0, 150.0, 600.0)  # durations of the search: a place found is then tried for all
-_BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a displaced rate comes back: octaves
-# A displaced rate, tried with a length half an octave from its own, keeps this share of its size over error.
-_CANDIDATES = 0.5**0.25
-_MARGIN = 1.2  # beyond chance: memories of the temperature leave kinks that no noise makes; chosen on recordings
+_BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a departure comes back: octaves
+_MARGIN = 1.25  # beyond chance: memories of the temperature leave kinks that no noise makes; chosen on recordings
 _KINDS = 4.0  # kinds of change, as looks: shapes of one kind are nearly one
 _INDEPENDENT = 5.0  # cells to a degree of freedom of a scale from a median of what is correlated
 _LEAST_CELLS = 60  # beside the columns that are fitted: fewer do not show what noise makes
@@ -82,15 +78,14 @@ class Change:
 
     Attributes:
         run: Number of the run.
-        kind: A step is over within 30 s or one row. A displaced rate comes back.
-        time_s: Of a step its first row behind, of a transition its middle, of a drift its beginning, of a displaced
-            rate its first row; 95 % limits, for a transition with its duration.
+        kind: A step is over within 30 s or one row.
+        time_s: Of a step its first row behind, of a transition its middle, of a drift its beginning; 95 % limits, for
+            a transition with its duration.
         duration_s: Of a transition, else 0.
         size: deg/h, of a drift deg/h each hour, of a gain the factor; 95 % limits.
         sigmas: Size over its standard error.
         gap_s: Length of the gap in the rows that it falls into, else 0.
         restarts: True if the gyro was switched on anew in that gap.
-        back_s: Of a displaced rate the first row behind it, with 95 % limits; None for the other kinds.
     """
 
     run: int
@@ -101,7 +96,6 @@ class Change:
     sigmas: float
     gap_s: float = 0.0
     restarts: bool = False
-    back_s: ValueWithLimits | None = None
 
     def falls_into(self, gap_s: tuple[float, float]) -> bool:
         """Test whether it happened while rows were missing; `gap_s`: times of the rows on both sides of the gap."""
@@ -110,27 +104,16 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class _At:
-    """A change as the search has it: beginning (s), duration (s), and the step by which a displaced rate comes back."""
+    """A change as the search has it: beginning (s), duration (s)."""
 
     run: int
     kind: RateChangeKind
     begin_s: float
     duration_s: float = 0.0
-    back: _At | None = None
 
     @property
     def middle_s(self) -> float:
         return self.begin_s + 0.5 * self.duration_s
-
-    @property
-    def steps(self) -> tuple[_At, ...]:
-        """The two steps of a displaced rate; else the change."""
-        return (self,) if self.back is None else (replace(self, kind="step", back=None), self.back)
-
-    def is_near(self, time_s: FloatArray | float, within_s: float) -> BoolArray:
-        """Test which times are near the change, or near a step of it."""
-        near = [np.abs(np.asarray(time_s) - one.middle_s) <= within_s for one in self.steps]
-        return np.asarray(np.any(near, axis=0))
 
     def columns(self, time_s: FloatArray, cell_s: float, curve: FloatArray) -> list[FloatArray]:
         """Return what a change of size 1 adds to cells with these means of time; of a gain first its own step.
@@ -141,8 +124,7 @@ class _At:
         if self.kind == "gain":
             behind = np.asarray(time_s >= self.begin_s, dtype=np.float64)
             return [behind, curve * behind]
-        column = self.column(time_s - self.begin_s, cell_s)
-        return [column if self.back is None else column - self.back.columns(time_s, cell_s, curve)[0]]
+        return [self.column(time_s - self.begin_s, cell_s)]
 
     def column(self, since: FloatArray, cell_s: float) -> FloatArray:
         """Return what a step, a transition or a drift of size 1 adds to cells at these times since its beginning, s."""
@@ -173,12 +155,12 @@ def changes_in_cells(cells: Sequence[RunCells], rows_of: Callable[[int], RowArra
     knots_c, noise = knots_and_noise(coarse)
     found: list[_At] = []
     curves: list[FloatArray] = [np.zeros((2, 1))] * len(fine)
-    for share in (_CANDIDATES, 1.0):
+    for _ in range(2):
         if found:
             beside = [_columns(one, k, found, curves) for k, one in enumerate(coarse)]
             noise, _ = likeliest_noise(Regression(coarse, maps_of(coarse, knots_c)), beside, noise)
         regression = Regression(fine, maps_of(fine, knots_c))
-        search = _Search(regression.white(noise.in_cells(min(one.cell_s for one in fine))), curves, share)
+        search = _Search(regression.white(noise.in_cells(min(one.cell_s for one in fine))), curves)
         found = search.found(found)
         if not found:
             return []
@@ -187,6 +169,25 @@ def changes_in_cells(cells: Sequence[RunCells], rows_of: Callable[[int], RowArra
     gains = [one for one in known if one.kind == "gain"]
     kept = [one for one in known if one in gains or not any(_within(one, gain) for gain in gains)]
     return sorted(kept, key=lambda one: (one.run, one.time_s[0]))
+
+
+def paired(changes: Sequence[Change]) -> Iterator[tuple[Change, Change | None]]:
+    """Yield the changes of a run; a step that comes back with the step that takes it back."""
+    k = 0
+    while k < len(changes):
+        one, back = changes[k], changes[k + 1] if k + 1 < len(changes) else None
+        comes_back = one.gap_s == 0.0 and back is not None and back.gap_s == 0.0 and _undoes(one, back)
+        yield one, back if comes_back else None
+        k += 2 if comes_back else 1
+
+
+def _undoes(one: Change, back: Change) -> bool:
+    """Test whether the second step takes the first one back, by their intervals."""
+    if {one.kind, back.kind} - {"step", "transition"}:
+        return False
+    low, high = sorted((-back.size[1], -back.size[2]))
+    own_low, own_high = sorted(one.size[1:])
+    return one.size[0] * back.size[0] < 0.0 and low <= own_high and own_low <= high
 
 
 def _within(one: Change, gain: Change) -> bool:
@@ -230,19 +231,11 @@ class _Looked:
 class _Search:
     """Runs with the noise that their changes are judged against."""
 
-    def __init__(self, runs: WhiteRuns, curves: list[FloatArray], share: float) -> None:
-        """Keep the runs; what noise makes of each shape is estimated when they are first looked at.
-
-        Args:
-            runs: Runs with whitened noise.
-            curves: Times and the map along each run, shape (2, n); the search fits them anew in this list.
-            share: Changes are returned from this share of the size on that makes one clear.
-        """
+    def __init__(self, runs: WhiteRuns, curves: list[FloatArray]) -> None:
         self._runs, self._cells, self._curves = runs, runs.regression.cells, curves
         self._looks = _KINDS * sum(len(one) for one in self._cells)
         chance = -float(stdtrit(self._looks / _KINDS / _INDEPENDENT, FALSE_ALARMS / 2.0 / self._looks))
-        self._limit = share * _MARGIN * chance
-        self._least = min(_CANDIDATES / share, 1.0) * self._limit  # at a place of the search, to be placed anew
+        self._limit = _MARGIN * chance
         # What noise makes of a change of size over error 1: of each shape, and how much more of each run
         self._scale: dict[_Tried, float] = {}
         self._louder: list[float] = []
@@ -260,7 +253,7 @@ class _Search:
             new = list(self._clearest(found))
             before = set(found)
             for gain in [at for at in new if at.kind == "gain"]:  # its own step goes with it
-                found = [at for at in found if at.run != gain.run or not at.is_near(gain.begin_s, _AROUND_S)]
+                found = [at for at in found if at.run != gain.run or abs(at.middle_s - gain.begin_s) > _AROUND_S]
             for run in sorted({at.run for at in new}):
                 found = self._placed_anew(run, found + [at for at in new if at.run == run])
             if before == set(found):
@@ -292,7 +285,7 @@ class _Search:
         return self._runs.fit([_columns(one, k, changes, self._curves) for k, one in enumerate(self._cells)])
 
     def _clearest(self, found: Sequence[_At]) -> Iterator[_At]:
-        """Yield the clearest change of each run if it is clear, or may be when its length is fitted."""
+        """Yield the clearest change of each run if it is clear; both steps of a departure that comes back."""
         for k, looked in enumerate(self._measure(found)):
             if sum(at.run == k for at in found) >= _MOST:
                 continue
@@ -300,19 +293,19 @@ class _Search:
             far = np.abs([z / (self._louder[k] * self._scale[shape]) for shape, z in looked.sizes.items()])
             for at in found:
                 if at.run == k:
-                    far[:, at.is_near(self._cells[k].time_s, self._separation_s(k))] = 0.0
+                    far[:, np.abs(self._cells[k].time_s - at.middle_s) <= self._separation_s(k)] = 0.0
             gain = self._clearest_gain(looked, k, found)
             if gain is not None and gain[0] > float(far.max()) ** 2 + self._limit:
                 yield gain[1]
                 continue
             s, place = np.unravel_index(int(np.argmax(far)), far.shape)
-            if far[s, place] > self._least:
-                kind, length = tried[s]
+            if far[s, place] > self._limit:
                 cells = self._cells[k]
                 begin = float(cells.time_s[place]) - 0.5 * cells.cell_s
-                if kind == "displaced":
-                    end = begin + round(length / cells.cell_s) * cells.cell_s
-                    yield _At(k, "displaced", begin, back=_At(k, "step", end))
+                kind, length = tried[s]
+                if kind == "back":
+                    yield _At(k, "step", begin)
+                    yield _At(k, "step", begin + round(length / cells.cell_s) * cells.cell_s)
                 elif kind == "drift":
                     yield _At(k, "drift", begin + 0.5 * cells.cell_s)
                 else:
@@ -320,8 +313,8 @@ class _Search:
 
     def _differ(self, one: _At, other: _At) -> bool:
         """Test whether two changes of a run are distinct."""
-        near = any(one.is_near(step.middle_s, self._separation_s(one.run)) for step in other.steps)
-        return not near or {one.kind, other.kind} == {"gain", "drift"}
+        apart = abs(one.middle_s - other.middle_s) > self._separation_s(one.run)
+        return apart or {one.kind, other.kind} == {"gain", "drift"}
 
     def _separation_s(self, run: int) -> float:
         """Least separation of two changes, s: nearer ones are one."""
@@ -372,7 +365,7 @@ class _Search:
             before = list(own)
             for k, at in enumerate(before):
                 own[k] = self._best(at, self._beside(fit, own[:k] + own[k + 1 :]))
-            own = self._one_or_two(self._at_steps(fit, own), fit)
+            own = self._at_steps(fit, own)
             if before == own:
                 break
         while own:
@@ -395,44 +388,12 @@ class _Search:
                     return self._at_steps(fit, [*rest, moved])
         return own
 
-    def _one_or_two(self, own: list[_At], fit: RunFit) -> list[_At]:
-        """Return the changes of a run, two steps as one displaced rate or the reverse by Schwarz's criterion (BIC).
-
-        One size less is estimated if the rate comes back to where it was. Over a gap it may have moved by itself, so
-        steps in gaps remain two.
-        """
-        for one in [at for at in own if at.kind == "displaced"]:
-            rest = [at for at in own if at is not one]
-            if self._are_two(one.steps, one, self._beside(fit, rest)):
-                own = [*rest, *one.steps]
-        steps = sorted((at for at in own if at.kind == "step"), key=lambda at: at.begin_s)
-        for first, second in pairwise(steps):
-            one = replace(first, kind="displaced", back=second)
-            if first in own and second in own:
-                rest = [at for at in own if at not in (first, second)]
-                if not self._are_two((first, second), one, self._beside(fit, rest)):
-                    own = [*rest, one]
-        return own
-
-    def _are_two(self, steps: Sequence[_At], one: _At, fit: RunFit) -> bool:
-        """Test whether two steps say so much more than one displaced rate that their sizes must differ.
-
-        Args:
-            fit: Beside the other changes of the run.
-        """
-        if any(self._gap_at(step) > 0.0 for step in steps):
-            return True
-        both = self._alone(fit, steps[0]) + self._alone(self._beside(fit, steps[:1]), steps[1])
-        return both - self._alone(fit, one) > float(np.log(len(self._cells[one.run])))
-
     def _best(self, at: _At, fit: RunFit) -> _At:
         """Return the likeliest place and duration of a change; `fit`: beside the other changes of the run.
 
         Of steps and transitions it is what is more likely, each of both kinds being as likely beforehand and all
         durations of a kind alike; a drift where it is nearly as likely as they are.
         """
-        if at.back is not None:
-            return self._best_ends(at, fit)
         cells = self._cells[at.run]
         reach = _HOUR_S if at.kind in ("drift", "gain") else max(_AROUND_S, at.duration_s, 3.0 * cells.cell_s)
         near = cells.time_s[np.abs(cells.time_s - at.middle_s) <= reach]
@@ -470,28 +431,6 @@ class _Search:
         mean = [np.mean([np.exp(0.5 * (gain - most)) for gain, _ in kind]) for kind in (over, lasting) if kind]
         steps = len(mean) == 1 or mean[0] >= mean[1]
         return max(over if steps else lasting, key=lambda pair: pair[0])[1]
-
-    def _best_ends(self, at: _At, fit: RunFit) -> _At:
-        """Return the likeliest beginning and end of a displaced rate, one after the other."""
-        cells = self._cells[at.run]
-        for _ in range(_ROUNDS):
-            before = at
-            for end in (False, True):
-                assert at.back is not None
-                least_s = max(self._separation_s(at.run), 2.0 * cells.cell_s)
-                length = at.back.middle_s - at.middle_s
-                reach = max(_AROUND_S, (_CANDIDATES**-2 - 1.0) * length)
-                shifts = np.arange(-reach, reach + cells.cell_s, cells.cell_s)
-                every = max(len(shifts) // _PLACES, 1)
-                between = cells.cell_s * np.arange(1.0 - every, every)
-                for tried_s in (shifts[::every], between, cells.cell_s * np.array(_PARTS)):
-                    kept = tried_s[(length + tried_s if end else length - tried_s) >= least_s]
-                    moved = [_shifted(at, float(s), end) for s in kept]
-                    if moved:
-                        at = moved[int(np.argmax(self._gains(fit, moved)))]
-            if at == before:
-                break
-        return at
 
     def _best_gain(self, at: _At, places_s: FloatArray, fit: RunFit) -> _At:
         """Return the likeliest of a change of gain and the same at other places."""
@@ -544,7 +483,6 @@ class _Search:
         inner, energy = self._amplitude(of_run, at)
         size, error = inner / energy, white / float(np.sqrt(energy))
         kind, duration, gap_s = at.kind, 0.0, self._gap_at(at) if at.kind == "step" else 0.0
-        back: ValueWithLimits | None = None
         if gap_s > 0.0:
             noise = self._runs.noise
             error = float(np.hypot(error, white * np.sqrt(noise.level * gap_s / noise.cell_s)))
@@ -554,12 +492,9 @@ class _Search:
         elif kind in ("drift", "gain"):
             time = self._begins(at, of_run)
         else:
-            near, around = rows[2] - np.interp(rows[0], cells.time_s, fit.curve(at.run)), _NEAR_CELLS * cells.cell_s
-            if at.back is not None:
-                around = min(around, at.back.middle_s - at.middle_s)
-                back = _placed(at.back, near, rows[0], around)
-            time = _placed(at, near, rows[0], around)
-            if kind == "step" and at.duration_s > _over_s(cells):
+            near = rows[2] - np.interp(rows[0], cells.time_s, fit.curve(at.run))
+            time = _placed(at, near, rows[0], _NEAR_CELLS * cells.cell_s)
+            if at.duration_s > _over_s(cells):
                 kind, duration = "transition", at.duration_s
                 half = 0.5 * duration + cells.cell_s
                 time = at.middle_s, at.middle_s - half, at.middle_s + half
@@ -569,7 +504,7 @@ class _Search:
                 return None
             size += 1.0
         limits = size, size - NORMAL_95 * error, size + NORMAL_95 * error
-        return Change(at.run, kind, time, duration, limits, sigmas, gap_s, back_s=back)
+        return Change(at.run, kind, time, duration, limits, sigmas, gap_s)
 
     def _gap_at(self, at: _At) -> float:
         """Length of the gap in the rows that a change lies in, s; 0: none."""
@@ -589,16 +524,6 @@ class _Search:
         gains = self._gains(fit, [replace(at, begin_s=float(s)) for s in near])
         likely = near[gains >= gains.max() - (_PLACED_95 if at.kind == "gain" else CHI2_95_ONE)]
         return float(near[int(np.argmax(gains))]), float(likely[0]) - 2.0 * cell_s, float(likely[-1]) + cell_s
-
-
-def _shifted(at: _At, by_s: float, end: bool) -> _At:
-    """Return a displaced rate whose end, or whose beginning, is another time."""
-    assert at.back is not None
-    return (
-        replace(at, back=replace(at.back, begin_s=at.back.begin_s + by_s))
-        if end
-        else replace(at, begin_s=at.begin_s + by_s)
-    )
 
 
 def _across_gap(at: _At, rows: RowArrays, around_s: float) -> ValueWithLimits:
@@ -680,7 +605,7 @@ def _shapes(n: int, cell_s: float) -> list[_Shape]:
     for length in _BACK_S:
         behind = round(length / cell_s)
         if 2 <= behind < n:
-            values["displaced", length] = np.asarray(np.arange(n) < behind, dtype=np.float64)
+            values["back", length] = np.asarray(np.arange(n) < behind, dtype=np.float64)
     values["drift", 0.0] = np.arange(0.0, n) * cell_s / _HOUR_S
     found = []
     for tried, shape in values.items():

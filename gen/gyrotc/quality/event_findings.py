@@ -12,7 +12,7 @@ from typing import Any
 from ..recordings.records import Dataset, Mark, Run, joined_runs
 from ..results.base import Finding
 from ..results.rows import STATED, LeftOutRows, RowsCount, RowsUsed
-from .changes import Change
+from .changes import Change, paired
 from .curves import curve_findings
 from .findings import ValueWithLimits, finding, run_facts
 from .judgement import Judged, Judgement, LeftOut, judge
@@ -293,15 +293,15 @@ def _stretches(judgement: Judgement) -> Iterator[LeftOutRows]:
 
 
 def _changes(judgement: Judgement) -> Iterator[Finding]:
-    """Yield a finding for each change."""
+    """Yield a finding for each change; a step that comes back is one."""
     run, (first_s, last_s) = judgement.run, judgement.span_s
     end_s = last_s + run.row_period_s
-    for one in judgement.changes:
-        if one.back_s is not None:
-            out = (one.time_s[1], one.back_s[2] + run.row_period_s)
+    for one, back in paired(judgement.changes):
+        if back is not None:
+            out = (one.time_s[1], back.time_s[2] + run.row_period_s)
             text = (
                 f"The rate of {run.file} steps by {one.size[0]:+.3g} deg/h at {one.time_s[0]:g} s and comes back at "
-                f"{one.back_s[0]:g} s, whatever the temperature is. What lies between ({_hours(*out)}) does not reach "
+                f"{back.time_s[0]:g} s, whatever the temperature is. What lies between ({_hours(*out)}) does not reach "
                 "the fit: find out what happened then."
             )
             yield finding("step_and_recover", text, run, time_s=one.time_s, size=(one.size, "deg/h"), leave_out=[out])

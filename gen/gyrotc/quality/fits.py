@@ -28,9 +28,7 @@ RowArrays = tuple[FloatArray, FloatArray, FloatArray]
 
 _KNOTS_C = (5.0, 2.5, 1.25)  # between knots of the map: finer ones only where the recordings say so
 _LEAST_SPAN_C = 1.0  # the temperature moves less: a level and a trend say all of it
-# Windows of dT/dt. With a fine sensor the short one follows the corners of a programme; with a resolution of 0.1 C only
-# the long one is of use, where that makes an error of 0.01 C/min.
-_SLOPES_S = (60.0, 300.0)
+_SLOPE_S = 300.0  # over which dT/dt is taken: a resolution of 0.1 C makes 0.01 C/min of it
 _WARM_UP_S = (300.0, 1000.0, 3000.0)  # time constants of a level that settles after power-on
 _GAP_CELLS = 3.0  # without rows: the next cell comes behind a gap
 LONGEST_GAP_S = 3000.0  # beyond it a gyro may drift by more than its noise says
@@ -433,9 +431,9 @@ def maps_of(cells: Sequence[RunCells], knots_c: float) -> list[FloatArray]:
     for one in cells:
         x = np.clip(one.temperature_c, low, high)
         pieces = cubic_splines(x, knots)[:, 1:].T  # with the first they add up to a level
-        slope, u = np.gradient(one.temperature_c, one.time_s), (x - 0.5 * (low + high)) / (high - low)
-        quick, r = (60.0 * running_mean(slope, max(round(window / one.cell_s), 1)) for window in _SLOPES_S)
-        found.append(np.concatenate([pieces, [quick, quick * u, r, r * u, r * u * u, r * np.abs(r), r * r]]))
+        slope = running_mean(np.gradient(one.temperature_c, one.time_s), max(round(_SLOPE_S / one.cell_s), 1))
+        r, u = 60.0 * slope, (x - 0.5 * (low + high)) / (high - low)
+        found.append(np.concatenate([pieces, [r, r * u, r * u * u, r * np.abs(r), r * r]]))
     return found
 
 

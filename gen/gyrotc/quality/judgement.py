@@ -19,7 +19,7 @@ from ..common.metrics import quantile_of_parts
 from ..common.statistics import NORMAL_95
 from ..recordings.records import Dataset, Rows, Run, joined_runs
 from ..recordings.records import inside as in_limits
-from .changes import Change, cell_length, changes_in_cells
+from .changes import Change, cell_length, changes_in_cells, paired
 from .curves import curve_findings
 from .fits import RowArrays, RunCells, cells_of_means
 from .jumps import jumps
@@ -181,16 +181,17 @@ def _with_changes(judgement: Judgement, changes: tuple[Change, ...], time_s: Flo
     changes = tuple(
         replace(one, restarts=one.kind == "step" and any(one.falls_into(gap) for gap in gaps)) for one in changes
     )
-    for change in changes:
-        low, high = change.time_s[1], (change.back_s or change.time_s)[2]
+    for change, back in paired(changes):
+        low, high = change.time_s[1], change.time_s[2] if back is None else back.time_s[2]
         first, end = np.searchsorted(time_s, (low, high), side="left").tolist()
         end = min(end + 1, len(time_s))
         kind: EventKind = "restart" if change.restarts else change.kind
         sigma = (change.size[2] - change.size[1]) / (2.0 * NORMAL_95)
         odds = 0.5 * change.sigmas**2 - cost_of(float(judgement.read))
-        why = "rate displaced" if change.kind == "displaced" else ""
-        if why:
-            _mark(reason, slice(first, end), why)
+        if back is not None:
+            kind = "displaced"
+            _mark(reason, slice(first, end), "rate displaced")
+        why = "rate displaced" if back is not None else ""
         span = (float(time_s[first]), float(time_s[end - 1]))
         events.append(Event(kind, "rate", (first, end), span, change.size[0], sigma, odds, why))
     return replace(

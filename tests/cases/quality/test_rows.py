@@ -34,18 +34,15 @@ def sound(rng: np.random.Generator, row_s: float, *, walk: bool = False) -> tupl
     return time, block + 0.01 * rng.standard_normal(time.size), rate
 
 
-def run_of(time: Array, temperature: Array, rate: Array, name: str = "a.csv") -> Run:
+def judged(time: Array, temperature: Array, rate: Array) -> Judgement:
     rows = Rows(time, temperature, rate, {})
     period = float(np.median(np.diff(time)))
-    return Run(
-        file=name, path=Path(name), sha256=name, role="train", environment="", started=None, power_on_s=None,
+    run = Run(
+        file="a.csv", path=Path("a.csv"), sha256="", role="train", environment="", started=None, power_on_s=None,
         from_s=None, to_s=None, exclude=(), row_period_s=period, n_rows=len(time), earth=None,
         pulse_weight_arcsec=None, reader=lambda: rows,
     )  # fmt: skip
-
-
-def judged(time: Array, temperature: Array, rate: Array) -> Judgement:
-    return judge_runs([run_of(time, temperature, rate)]).runs[0]
+    return judge_runs([run]).runs[0]
 
 
 def left_out(judgement: Judgement, count: int) -> NDArray[np.bool_]:
@@ -196,35 +193,3 @@ def test_a_displaced_rate_is_left_out_in_a_test_run_too() -> None:
     rate[2000:2060] += 0.02
     judgement = judged(time, temperature, rate)
     assert left_out(judgement, len(rate))[2002:2058].all()
-
-
-@pytest.mark.parametrize("length_s", [200.0, 700.0, 2000.0])
-def test_a_rate_that_is_displaced_by_twelve_sigma_of_its_mean_is_one_event_of_its_run(length_s: float) -> None:
-    """Neither of its two steps needs to be clear by itself; lengths are between those that the search tries."""
-    count, found = round(length_s / 10.0), []
-    for k in range(5):
-        runs = [sound(np.random.default_rng([SEED, k, number]), 10.0) for number in range(4)]
-        rate = runs[0][2]
-        first = round((0.35 + 0.06 * k) * len(rate))
-        rate[first : first + count] += 12.0 * 7e-3 / np.sqrt(10.0 * count) * (-1) ** k
-        judgements = judge_runs([run_of(*one, f"{number}.csv") for number, one in enumerate(runs)]).runs
-        events = [(number, one) for number, of_run in enumerate(judgements) for one in of_run.events]
-        found += [number == 0 and one.kind == "displaced" for number, one in events]
-        ends = [one.rows for number, one in events if number == 0]
-        assert all(abs(low - first) + abs(high - first - count) < 0.5 * count + 8 for low, high in ends)
-    assert found.count(True) >= 4  # of one the temperatures explain two thirds
-    assert found.count(False) == 0
-
-
-def test_a_rate_that_is_displaced_for_a_day_is_left_out_from_end_to_end() -> None:
-    """Its ends are placed as well as those of a short one."""
-    rng = np.random.default_rng([5, 2])
-    time = np.arange(0.0, 3600.0 * 50, 10.0)
-    temperature = 15.0 + 30.0 * np.sin(time / 9000.0)
-    block = temperature + 0.01 * rng.standard_normal(time.size)
-    rate = 0.01 * np.tanh(temperature / 30.0) + 7e-3 / np.sqrt(10.0) * rng.standard_normal(time.size)
-    first, end = 2426, 14320
-    rate[first:end] += 0.006
-    [event] = judged(time, block, rate).events
-    assert event.kind == "displaced"
-    assert first - 8 <= event.rows[0] <= first and end <= event.rows[1] <= end + 8
