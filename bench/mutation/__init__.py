@@ -39,8 +39,10 @@ FAULTS, QUICK_FAULTS = 300, 20
 AIM = 0.85
 _SEED = 1
 _PYTEST = (".venv/bin/python", "-m", "pytest", "-x", "-q", "-p", "no:randomly", "-p", "no:cacheprovider")
-#: Tests with a fault are stopped after so many times what they took without it, and a minute: it is found.
-_LIMIT = 10.0
+#: A fault is found if the tests with it take longer than so many times what they took without it ...
+_MAX_SLOWDOWN = 10.0
+#: ... and this, s, for the start of pytest and a machine that is busy.
+_START_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +147,8 @@ def _there(folder: Path, pattern: str) -> list[Path]:
 
 
 @dataclass
-class _Map:
-    """Which tests execute which lines; each test file is followed once, when it is first asked for.
+class _TestsByLine:
+    """Tests with the lines that they execute; each test file is followed once, when it is first asked for.
 
     Attributes:
         copy: The sources without a fault.
@@ -195,7 +197,7 @@ def _tried(
     faults = drawn(modules, count, np.random.default_rng([seed, *name.encode()]))
     missed: list[Fault] = []
     with tempfile.TemporaryDirectory(prefix="gyrotc-mutation-") as folder, ThreadPoolExecutor(workers) as threads:
-        reach, lock = _Map(copy_of_sources(Path(folder, "whole"))), threading.Lock()
+        by_line, lock = _TestsByLine(copy_of_sources(Path(folder, "whole"))), threading.Lock()
         copies: queue.SimpleQueue[Path] = queue.SimpleQueue()
         for number in range(workers):
             copies.put(copy_of_sources(Path(folder, str(number))))
@@ -206,7 +208,7 @@ def _tried(
             try:
                 for files in stages:
                     with lock:
-                        tests = reach.reaching(fault, files)
+                        tests = by_line.reaching(fault, files)
                     begun = time.monotonic()
                     failed = _finding(copy, fault, tests)
                     spent += time.monotonic() - begun
@@ -236,7 +238,7 @@ def _finding(copy: Path, fault: Fault, tests: dict[str, float]) -> str:
         return ""
     with planted(copy, fault):
         try:
-            return _pytest(copy, list(tests), _LIMIT * sum(tests.values()) + 60.0)
+            return _pytest(copy, list(tests), _MAX_SLOWDOWN * sum(tests.values()) + _START_S)
         except subprocess.TimeoutExpired:
             return "it never ends"
 

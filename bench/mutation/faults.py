@@ -66,11 +66,8 @@ def drawn(modules: Sequence[Path], count: int, rng: np.random.Generator) -> list
 
 
 @contextmanager
-def planted(copy: Path, fault: Fault | None) -> Iterator[None]:
+def planted(copy: Path, fault: Fault) -> Iterator[None]:
     """Plant a fault in a copy of the sources for a block."""
-    if fault is None:
-        yield
-        return
     path = copy / fault.file
     whole = path.read_text("utf-8")
     path.write_text(fault.text, "utf-8")

@@ -13,7 +13,8 @@ import sys
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
@@ -67,8 +68,9 @@ class Reach:
 
 
 _REACH = Reach()
-_TESTS: dict[str, dict[str, Any]] = {}
-_SHARED: Lines = defaultdict(set)
+_SECONDS: dict[str, float] = defaultdict(float)  # by test
+_LINES: dict[str, Lines] = defaultdict(lambda: defaultdict(set))  # by test
+_LINES_OF_FIXTURES: Lines = defaultdict(set)
 
 
 def pytest_configure() -> None:
@@ -79,31 +81,37 @@ def pytest_configure() -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
-    """Gather what fixtures execute."""
-    lines = _REACH.begin()
-    begun = time.monotonic()
-    try:
+    """Follow the fixtures of a test."""
+    with _followed(item, _LINES_OF_FIXTURES):
         return (yield)
-    finally:
-        _TESTS[item.nodeid] = {"seconds": time.monotonic() - begun, "lines": {}}
-        for name, numbers in lines.items():
-            _SHARED[name] |= numbers
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
-    """Gather what a test executes."""
-    lines = _REACH.begin()
+    """Follow a test."""
+    with _followed(item, _LINES[item.nodeid]):
+        return (yield)
+
+
+@contextmanager
+def _followed(item: pytest.Item, lines: Lines) -> Iterator[None]:
+    """Add to `lines` what is executed within the block, and to the seconds of the test what it takes."""
+    executed = _REACH.begin()
     begun = time.monotonic()
     try:
-        return (yield)
+        yield
     finally:
-        _TESTS[item.nodeid]["seconds"] += time.monotonic() - begun
-        _TESTS[item.nodeid]["lines"] = {name: sorted(numbers) for name, numbers in lines.items()}
+        _SECONDS[item.nodeid] += time.monotonic() - begun
+        for name, numbers in executed.items():
+            lines[name] |= numbers
 
 
 def pytest_sessionfinish() -> None:
     """Write the file."""
     sys.settrace(None)
-    shared = {name: sorted(numbers) for name, numbers in _SHARED.items()}
-    Path(os.environ[OUTPUT]).write_text(json.dumps({"tests": _TESTS, "fixtures": shared}), "utf-8")
+    tests = {test: {"seconds": seconds, "lines": _sorted(_LINES[test])} for test, seconds in _SECONDS.items()}
+    Path(os.environ[OUTPUT]).write_text(json.dumps({"tests": tests, "fixtures": _sorted(_LINES_OF_FIXTURES)}), "utf-8")
+
+
+def _sorted(lines: Lines) -> dict[str, list[int]]:
+    return {name: sorted(numbers) for name, numbers in lines.items()}
