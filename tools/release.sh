@@ -31,24 +31,24 @@ prepare() {
   echo "release: look at it, run the tests, then: git commit -am 'Release $1' && git tag -a v$1 -m 'gyrotc $1' && make release TAG=v$1"
 }
 
-# older COMMIT FOLDER: the records of FOLDER that were measured with other sources than those of COMMIT, each with the commit
-# that it states. A record without one is made again and compared by its own command.
-older() {
-  local record measured same
+# outdated COMMIT FOLDER: the records of FOLDER that were measured with other sources than those of COMMIT, each with the
+# commit that it states. A record without one is made again and compared by its own command.
+outdated() {
+  local record measured changes
   for record in "$2"/docs/results/*.json; do
     [ -e "$record" ] || continue
     measured=$(sed -n 's/.*"commit": "\([^"]*\)".*/\1/p' "$record" | head -n 1)
     [ -n "$measured" ] || continue
-    same=
-    if [[ $measured != *+ ]] && git cat-file -e "$measured^{commit}" 2>/dev/null; then
-      [ -n "$(git diff -I'^version = "' -I'^__version__ = "' -I'^#define GTC_VERSION_' "$measured" "$1" -- gen libc include)" ] || same=1
+    # git fails on what is no commit here: one with a `+`, one that a clone without history does not have
+    if ! changes=$(git diff -I'^version = "' -I'^__version__ = "' -I'^#define GTC_VERSION_' "$measured" "$1" -- gen libc include 2>/dev/null) ||
+      [ -n "$changes" ]; then
+      echo "$(basename "$record" .json) ($measured)"
     fi
-    [ -n "$same" ] || echo "$(basename "$record" .json) ($measured)"
   done
 }
 
 archive() {
-  local commit=HEAD version out
+  local commit=HEAD version out records
   if [ $# -gt 0 ] && [ "$1" != --sdist ]; then
     [[ $1 =~ ^v$number$ ]] || fail "'$1' is no tag of a release; expected v and three numbers, as v0.2.0"
     git rev-parse -q --verify "refs/tags/$1" >/dev/null || fail "there is no tag $1"
@@ -69,7 +69,7 @@ archive() {
     grep -qE "^## ${version//./\\.} \([0-9]{4}-[0-9]{2}-[0-9]{2}\)$" "$sources/CHANGELOG.md" ||
       fail "CHANGELOG.md of $commit has no dated section $version"
   fi
-  records=$(older "$commit" "$sources" | paste -sd, | sed 's/,/, /g')
+  records=$(outdated "$commit" "$sources" | paste -sd, | sed 's/,/, /g')
   if [ -n "$records" ]; then
     records="records of other sources in gen, libc or include: $records; measure them again: make bench ONLY=NAME, make targets, make prove, make blind"
     [ "$commit" = HEAD ] || fail "$records"

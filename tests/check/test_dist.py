@@ -151,16 +151,17 @@ def clone(tmp_path: Path) -> Path:
 
 
 def test_from_tag_to_archives(clone: Path) -> None:
-    """Prepared where nothing is set up yet; archives of the tag, packages by the tag's own generator."""
-    reported = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
-    assert "git tag -a v0.2.0" in reported
-    assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
+    """Measured, then prepared where nothing is set up yet; archives of the tag, packages by its own generator."""
     command = clone / "gen" / "gyrotc" / "cli" / "schema.py"
     command.write_text(
         command.read_text("utf-8").replace("Print the JSON Schema of", "Print of the tag the JSON Schema of"), "utf-8"
     )
     _run("git", "commit", "-qam", "The command of the release", cwd=clone)
     _measured_with(clone, _run("git", "rev-parse", "--short=8", "HEAD", cwd=clone).strip())
+    _run("git", "commit", "-qam", "The records of the release", cwd=clone)
+    reported = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
+    assert "git tag -a v0.2.0" in reported
+    assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
     (clone / "libc" / "gtc_f32.c").write_text("not of the tag", "utf-8")
@@ -194,7 +195,7 @@ def _measured_with(folder: Path, commit: str) -> None:
 
 @pytest.mark.parametrize("path", ["gen/gyrotc/model.py", "libc/gtc_f32.c", "include/gtc.h"])
 def test_a_release_whose_records_are_of_other_sources_is_refused_by_their_names(clone: Path, path: str) -> None:
-    """The version may differ, and pages; a line of the sources may not."""
+    """A line of the sources may not differ; the version may, as the test above shows."""
     measured = _run("git", "rev-parse", "--short=8", "HEAD", cwd=clone).strip()
     _measured_with(clone, measured)
     with (clone / path).open("a", encoding="utf-8") as source:
