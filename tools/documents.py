@@ -89,7 +89,10 @@ def shown(text: str) -> list[Shown]:
 
 
 def typed(text: str) -> Iterator[list[str]]:
-    """Yield the words of every command in the blocks of a page, run or only shown, without prompt and quotes."""
+    """Yield the words of each command in the blocks of a page, run or only shown, without prompt and quotes.
+
+    Lines that a command prints are not told from commands.
+    """
     for block in _FENCE.finditer(text):
         for line in block["body"].replace("\\\n", " ").splitlines():
             for part in re.split(r"&&|[;|]", line.strip().removeprefix("$ ").partition(" #")[0]):
