@@ -244,13 +244,11 @@ class Object:
     """A compiled source, and what was measured on it.
 
     Attributes:
-        name: Hash of what it was made of but for headers; empty where that cannot be determined.
         headers: SHA-256 of each header by its path, which is relative where it lies in the folder of headers.
         code: The file.
         graph: Who calls whom, and the stack of each function, as gcc writes it; empty where it was not asked for.
     """
 
-    name: str
     headers: tuple[tuple[str, str], ...]
     code: bytes
     symbols: tuple[Symbol, ...]
@@ -290,13 +288,12 @@ def shared_object(target: Target, source: Path, work: Path, *, include: Path, fr
         CheckFailed: The compiler refused.
     """
     name = "" if fresh else _name_of(target, source)
-    found = cache.kept(name, functools.partial(_object, name, include)) if name else None
+    found = cache.kept(name, functools.partial(_object, include)) if name else None
     if found is None:
         listing = target.model_copy(update={"flags": (*target.flags, "-MD")})
         (path,) = compile_objects(listing, [source], work, include=include)
         graph = path.with_suffix(".ci")
         found = Object(
-            name,
             tuple(_headers(path.with_suffix(".d"), source, include)),
             path.read_bytes(),
             tuple(symbols(target, path)),
@@ -320,7 +317,7 @@ def _content(found: Object) -> bytes:
     return canonical_json(measured) + b"\n" + found.code
 
 
-def _object(name: str, include: Path, content: bytes) -> Object | None:
+def _object(include: Path, content: bytes) -> Object | None:
     """Return the object that was kept, or None if one of its headers changed since."""
     line, _, code = content.partition(b"\n")
     measured = json.loads(line)
@@ -329,7 +326,7 @@ def _object(name: str, include: Path, content: bytes) -> Object | None:
         return None
     rows = tuple(Symbol(*row) for row in measured["symbols"])
     sound = code and type(measured["writable_bytes"]) is int and type(measured["graph"]) is str
-    return Object(name, headers, code, rows, measured["writable_bytes"], measured["graph"]) if sound else None
+    return Object(headers, code, rows, measured["writable_bytes"], measured["graph"]) if sound else None
 
 
 def _headers(listed: Path, source: Path, include: Path) -> Iterator[tuple[str, str]]:
@@ -343,7 +340,10 @@ def _headers(listed: Path, source: Path, include: Path) -> Iterator[tuple[str, s
 
 
 def _name_of(target: Target, source: Path) -> str:
-    """Name under which an object is kept; empty where compiler or processor cannot be determined."""
+    """Return the name under which an object is kept: a hash of all that it is made of except headers.
+
+    It is empty if compiler or processor cannot be determined.
+    """
     compiler = compiler_identity(target.compiler)
     processor = _processor() if "-march=native" in target.flags else "any"
     if not compiler or not processor:
@@ -388,7 +388,7 @@ def _bare_objects(target: Target) -> tuple[tuple[str, Object], ...]:
 
 
 def link(target: Target, objects: Sequence[Path], program: Path) -> None:
-    """Links objects, and the bare parts of the target, into a program.
+    """Link objects, and the bare parts of the target, into a program.
 
     Raises:
         CheckFailed: The linker refused.
