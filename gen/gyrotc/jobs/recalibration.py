@@ -18,14 +18,14 @@ from ..train.fitting import FitOptions
 from ..train.prior.earlier import EarlierPrior, posterior_of_result, widened
 
 
-def prior_from(folder: Path, dataset: Dataset, limits: Limits | None = None) -> EarlierPrior:
+def prior_from(folder: Path, dataset: Dataset, limits: Limits | None) -> EarlierPrior:
     """Return what an earlier result says of a unit today.
 
     Args:
         folder: What `gyrotc build` wrote of the same gyro.
         dataset: The recordings of the check run.
-        limits: Limits of the product, with the drift of the type; None: the earlier calibrations of the unit state
-            how far the bias may have moved since.
+        limits: Limits of the product; the drift of the type in them says how far the bias may have moved since, else
+            the earlier calibrations of the unit do.
 
     Raises:
         InputError: It is of another gyro, cannot be read, or is made from the same recordings.
@@ -56,9 +56,8 @@ def with_prior(options: FitOptions, dataset: Dataset, folder: Path | None, limit
     """Return options of a fit with the prior of an earlier result; unchanged if none is named.
 
     Raises:
-        InputError: As `refuse_together` and `prior_from`.
+        InputError: As `prior_from`.
     """
-    refuse_together(options, folder)
     if folder is None:
         return options
     return replace(options, prior=prior_from(folder, dataset, limits))
