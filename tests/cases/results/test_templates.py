@@ -1,7 +1,8 @@
-"""Templates that are compiled once, and again where what was kept is damaged."""
+"""Templates that are compiled once, and again if what was kept is damaged or of other programs."""
 
 from __future__ import annotations
 
+from importlib import metadata
 from pathlib import Path
 
 import jinja2
@@ -50,5 +51,14 @@ def test_a_template_of_another_python_is_compiled_again(compilations: list[str])
     first = _text()
     (kept,) = cache.folder().glob("*.template")
     cache.keep(kept.name, b"another magic number, then code")
+    assert _text() == first
+    assert compilations == ["footprint.c.j2"] * 2
+
+
+def test_a_template_of_another_jinja2_is_compiled_again(
+    compilations: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = _text()
+    monkeypatch.setattr(metadata, "version", lambda name: f"another {name}")
     assert _text() == first
     assert compilations == ["footprint.c.j2"] * 2
