@@ -92,7 +92,7 @@ NumericOption = Annotated[
     str | None,
     typer.Option(
         "--numeric",
-        help="Arithmetics, e.g. f32 or f32,q31; default: those of the limits file, else all.",
+        help="Arithmetics, e.g. f32 or f32,q31; default: all, in build those that the limits need.",
         autocompletion=completing(("f32", "q31", "f32,q31")),
     ),
 ]

@@ -4,8 +4,8 @@ A file is the SHA-256 of its name and content, followed by the content. Three th
 own (made with mode 0700; one that belongs to somebody else, or that others may write, is not used); the checksum finds
 damage and a content that lies under another name; and a reader takes nothing from a content but what it should hold.
 A file that does not fit is removed, and its content is computed again. `joblib.Memory` has no such protection: it
-unpickles whatever it finds. Compiled templates are code of Python, as its own `__pycache__` holds beside every module:
-whoever could change them could change those.
+unpickles whatever it finds. Objects and compiled templates are code that will run, so no reader can tell what they
+should hold: for them the first two have to be enough.
 """
 
 from __future__ import annotations

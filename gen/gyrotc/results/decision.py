@@ -23,8 +23,7 @@ def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool,
     """Return what to do next with a unit, one step.
 
     Code that failed a check comes first, then recordings that are worthless, then an arithmetic whose rounding is above
-    the noise. A diagnosis is made of the recordings that
-    are there, so it comes before any advice to record more.
+    the noise. A diagnosis is made of the recordings that are there, so it comes before any advice to record more.
 
     DATASET stands for the recordings, DIR for the result.
 
