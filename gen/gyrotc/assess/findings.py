@@ -12,7 +12,6 @@ noise floor comes from successive differences, so that slow structure raises bot
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -28,7 +27,7 @@ from ..recordings.records import Dataset
 from ..results.base import Finding
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
 from ..results.training import Training
-from ..tables.quantisation import rms_growth
+from ..tables.quantisation import rms_growth, rounding_bound_dph
 from ..train.noise import robust_sigma
 
 _LAGS = 10  # means: of 100 s a third of the shortest ramp of a chamber's cycle
@@ -138,7 +137,7 @@ def coarse_arithmetic(model: Model, table: Table) -> Iterator[Finding]:
     growth, floor_dph = rms_growth(model, table), model.noise_floor_dph
     if growth is None or floor_dph is None or growth <= RMS_OVER_FLOOR - 1.0:
         return
-    error_dph, constant_dph = floor_dph * math.sqrt((1.0 + growth) ** 2 - 1.0), model.fallback_dph
+    error_dph, constant_dph = rounding_bound_dph(model, table), model.fallback_dph
     if table.numeric == "q31":  # its digits are those of a unit that no rate changes
         why = f"the unit of its bias is 2^-{table.bias_frac_bits} deg/h"
         advice = "State a larger q31_bias_frac_bits in the limits file, or take the f32 table, and build again."

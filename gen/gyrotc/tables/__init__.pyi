@@ -17,6 +17,7 @@ from .quantisation import channels_of as channels_of
 from .quantisation import outside as outside
 from .quantisation import quantise as quantise
 from .quantisation import rms_growth as rms_growth
+from .quantisation import rounding_bound_dph as rounding_bound_dph
 from .record import RECORD as RECORD
 from .record import read_options as read_options
 from .runtime import SWITCHES as SWITCHES

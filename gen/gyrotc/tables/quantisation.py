@@ -40,7 +40,7 @@ from ..results.base import NUMERICS
 from . import f32, q31
 from .error_bounds import channel_error_dph, with_authority
 
-__all__ = ["NUMERICS", "N_PROBES", "Table", "outside", "quantise", "rms_growth", "with_probes"]
+__all__ = ["NUMERICS", "N_PROBES", "Table", "outside", "quantise", "rms_growth", "rounding_bound_dph", "with_probes"]
 
 _ROW = re.compile(r"RANGE\((.*?)\),(?:\s*/\* ([^*]*?) \*/)?$")
 _NAME = re.compile(r"^#define (GTC_\w+) (\d+)U?\b", re.MULTILINE)
@@ -305,13 +305,17 @@ def _quantised(known: _Known, numeric: str) -> Table:
 def rms_growth(model: Model, table: Table) -> float | None:
     """Return the share by which rounding can raise the RMS of a residual; None if the model states no noise floor.
 
-    An error of rounding is constant at a constant temperature, so averaging does not reduce it: the bounds of the map
-    and of the terms of channels are added, in squares, to the noise floor of means over the averaging time.
+    An error of rounding is constant at a constant temperature, so averaging does not reduce it: its bound is added, in
+    squares, to the noise floor of means over the averaging time.
     """
     if not model.noise_floor_dph:
         return None
-    bound_dph = table.error_bound_dph + channel_error_dph(model.for_tables(), table.numeric, table.bias_frac_bits)
-    return math.hypot(1.0, bound_dph / model.noise_floor_dph) - 1.0
+    return math.hypot(1.0, rounding_bound_dph(model, table) / model.noise_floor_dph) - 1.0
+
+
+def rounding_bound_dph(model: Model, table: Table) -> float:
+    """Return the bound of what rounding does to map and terms of channels, deg/h."""
+    return table.error_bound_dph + channel_error_dph(model.for_tables(), table.numeric, table.bias_frac_bits)
 
 
 _PART = 2**18  # rows that are looked at together: bounds memory
