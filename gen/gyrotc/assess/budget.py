@@ -304,12 +304,11 @@ def _unseen(evaluation: Evaluation, explained: float) -> Contribution | str:
     The excess of their mean square is known with an error, and it cannot be negative. Its expectation under both is
     what counts: it falls to nothing only where many means show that nothing is there.
     """
-    judged = evaluation.judged()
-    lasting = judged[1].lasting if judged and judged[0] != "train" else None
-    if judged is None or lasting is None:
-        why = "no recordings were left out"
-        if judged is not None and judged[0] != "train":  # too few means, or a result of an older gyrotc
-            why = f"no error that lasts is known of {PARTS[judged[0]]}"
+    name, pooled = evaluation.judged() or ("train", None)
+    lasting = pooled.lasting if pooled and name != "train" else None
+    if pooled is None or lasting is None:
+        # Of held-out recordings it is not known if their means are few, or if the result is of an older gyrotc.
+        why = "no recordings were left out" if name == "train" else f"no error that lasts is known of {PARTS[name]}"
         constant = evaluation.train.constant.rms_dph if evaluation.train else None
         if constant is None:
             return f"thermal history that was not trained: {why}"
@@ -323,7 +322,7 @@ def _unseen(evaluation: Evaluation, explained: float) -> Contribution | str:
         "unseen",
         "thermal history and rates that were not trained",
         math.sqrt(positive_mean(lasting.mean_square_dph2 - explained**2, lasting.standard_dph2)),
-        f"{judged[1].samples} means of {PARTS[judged[0]]}: what lasts for half an hour, beyond what the table states",
+        f"{pooled.samples} means of {PARTS[name]}: what lasts for half an hour, beyond what the table states",
         freedom=lasting.freedom,
         statistical=True,
     )

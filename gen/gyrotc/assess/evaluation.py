@@ -463,7 +463,7 @@ def _arrow(values: NDArray[Any]) -> pa.Array:
 
 
 def _means(columns: list[FloatArray], each: int) -> list[FloatArray]:
-    """Return means of every `each` rows of columns; rows in which the third is NaN count only among their like."""
+    """Return means of every `each` rows of columns, of the rows in which the third is known if there are any."""
     if each == 1:
         return columns
     starts = np.arange(0, columns[0].size, each)

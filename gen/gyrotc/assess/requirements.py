@@ -104,7 +104,7 @@ def _rows(facts: Sequence[RunFacts], test_rows: Sequence[RowsCount]) -> Requirem
             if f.saturated_rows
         ),
     ]
-    bad, kept = (sum(getattr(rows, name) for rows in test_rows) for name in ("bad", "kept"))
+    kept, bad = sum(rows.kept for rows in test_rows), sum(rows.bad for rows in test_rows)
     share = kept / (kept + bad) if kept + bad else 1.0
     usable = f"{share:.0%} of the rows of the test runs may be used" if test_rows else ""
     if reasons or share < _MIN_TESTABLE:

@@ -296,9 +296,9 @@ def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
 
 
 def _within_runs(stage: _Stage, pairs: Sequence[Point], size: int) -> Point | None:
-    """Return the best pair with the cause that the search finds within runs, beside one that is constant in each.
+    """Return the best pair of a cause that is constant in each run and the one that the search finds within runs.
 
-    Such a cause has no form within runs, so what is found there is not its imperfection, and the level of the search is
+    The first has no form within a run, so what is found there is not its imperfection, and the level of the search is
     enough.
     """
     (first,) = stage.chosen

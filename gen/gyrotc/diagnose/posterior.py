@@ -107,6 +107,6 @@ class Posterior:
 
     @property
     def is_chance(self) -> bool:
-        """True if nothing in the place is likelier than the chosen cause, and than something unnamed."""
+        """True if the hypothesis `NOTHING` is likelier than the chosen cause and than something unnamed."""
         share = self.probabilities
         return share.get(NOTHING, 0.0) > max(share[self.id], share.get(UNNAMED, 0.0))

@@ -192,7 +192,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int, cycle: Cycle | None
         posterior = attribution.posteriors[k]
         near, probabilities = posterior.remaining, posterior.probabilities
     else:
-        near, probabilities = cycle.rivals if k == 0 else (), None
+        near, probabilities = (cycle.rivals if k == 0 else ()), None
     rivals = tuple(dict.fromkeys(r.id for r in near))[:_MOST_EQUIVALENT]
     words = CATALOGUE[id].words
     named = NamedCause(

@@ -459,7 +459,7 @@ class VarianceSearch:
         s = self.structure
         usual, less = self.mean.copy(), self.mean.copy()
         if s.own:
-            less[: min(s.map_parameters, 3)] -= _LESS_MAP
+            less[: len(_PRIOR_OF_FEW)] -= _LESS_MAP
             less[s.map_parameters : -1] += _MORE_OWN
         usual[4], less[4] = np.log(_START_SCALES)
         return [usual, less]

@@ -1,4 +1,4 @@
-"""Cubic B-splines against those of scipy, which the commands do not import."""
+"""Cubic B-splines against those of `scipy.interpolate`."""
 
 from __future__ import annotations
 
