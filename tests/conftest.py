@@ -269,7 +269,7 @@ def _read_by(command: list[str]) -> str:
 def objects_compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What this process compiles twice from the same bytes with the same command is compiled once.
 
-    Builds of different gyros have the same `gtc_f32.c`, at which a compiler works for a second.
+    These are programs of board tests, and runtimes of joint tables. Objects with a list of headers are kept by gyrotc.
     """
     from gyrotc.verify import toolchain
 

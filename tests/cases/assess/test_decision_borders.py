@@ -320,10 +320,6 @@ def test_a_temperature_is_late_beyond_six_standard_errors_of_its_lag(place: int,
     assert found(0.95 * limit) == []
 
 
-def training_like(samples: int) -> Any:
-    return SimpleNamespace(noise_floor_dph=FLOOR, samples=samples, block_s=10.0, average_s=100.0)
-
-
 @pytest.mark.parametrize("excess", [-20.0, -3.0, -1.0, 0.0, 1.0, 3.0, 20.0])
 def test_unseen_history_counts_with_the_mean_excess_that_its_error_allows(
     excess: float, model_dict: dict[str, Any]
@@ -388,19 +384,12 @@ def unseen_of(model_dict: dict[str, Any], lasting: LastingError | None, sigma: f
 
 def unseen_part(model_dict: dict[str, Any], lasting: LastingError | None, sigma: float) -> Any:
     """Return the row of the budget for unseen history of test runs whose error lasts so much."""
-    figures = Statistics(mean_dph=0.0, std_dph=1e-3, rms_dph=1e-3, max_abs_dph=5e-3)
-    exam = Pooled(
-        before=figures,
-        constant=figures,
-        after=figures,
-        improvement=1.0,
-        improvement_about_zero=1.0,
-        samples=100,
-        lasting=lasting,
-    )
     made = evaluation_of([evaluated("exam"), evaluated("train")], sigma_rms_dph=sigma)
+    assert made.exam is not None
+    exam = made.exam.model_copy(update={"lasting": lasting})
     made = made.model_copy(update={"exam": exam, "train": made.exam})
-    budget = budget_of(Model.from_dict(model_dict), training_like(3000), made, None)
+    training: Any = SimpleNamespace(noise_floor_dph=FLOOR, samples=3000, block_s=10.0, average_s=100.0)
+    budget = budget_of(Model.from_dict(model_dict), training, made, None)
     (unseen,) = (one for one in budget.contributions if one.id == "unseen")
     return unseen
 

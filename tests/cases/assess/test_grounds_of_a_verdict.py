@@ -35,14 +35,18 @@ improvement = 1.5
 """
 
 
+def bias_dph(temperature: Any) -> Any:
+    return 0.6 * ((temperature - 20.0) / 20.0) ** 2 + 0.02 * temperature
+
+
 def rows_of(seed: int) -> Rows:
     """A triangle of temperature over 40 C in two and a half hours, a bias of 1 deg/h over it, and white noise."""
     rng = np.random.default_rng(seed)
     t = PERIOD_S * np.arange(ROWS)
     phase = t / t[-1]
     temperature = 40.0 * (1.0 - np.abs(2.0 * phase - 1.0)) + rng.normal(0.0, 0.005, ROWS)
-    bias = 0.6 * ((temperature - 20.0) / 20.0) ** 2 + 0.02 * temperature
-    return {"time_s": t, "temperature_c": temperature, "rate_dph": bias + rng.normal(0.0, SIGMA_DPH, ROWS)}
+    rate = bias_dph(temperature) + rng.normal(0.0, SIGMA_DPH, ROWS)
+    return {"time_s": t, "temperature_c": temperature, "rate_dph": rate}
 
 
 Runs = dict[str, tuple[str, Rows]]
@@ -89,9 +93,8 @@ def held_at(c: float, span_c: float) -> Callable[[Rows], Rows]:
 
     def change(rows: Rows) -> Rows:
         t = c + 0.5 * span_c * np.sin(np.linspace(0.0, 6.0 * np.pi, ROWS))
-        bias = 0.6 * ((t - 20.0) / 20.0) ** 2 + 0.02 * t
         noise = np.random.default_rng(99).normal(0.0, SIGMA_DPH, ROWS)
-        return rows | {"temperature_c": t, "rate_dph": bias + noise}
+        return rows | {"temperature_c": t, "rate_dph": bias_dph(t) + noise}
 
     return change
 
@@ -108,9 +111,8 @@ def goes_on(rows: Rows) -> Rows:
     """The recording goes on for seven times as long after the logger has died; what it repeats is right."""
     dead = 7 * ROWS
     time_s = rows["time_s"][-1] + PERIOD_S * np.arange(1, dead + 1)
-    last_c = rows["temperature_c"][-1]
-    bias = 0.6 * ((last_c - 20.0) / 20.0) ** 2 + 0.02 * last_c
-    after = {"time_s": time_s, "temperature_c": np.full(dead, last_c), "rate_dph": np.full(dead, bias)}
+    held_c = np.full(dead, rows["temperature_c"][-1])
+    after = {"time_s": time_s, "temperature_c": held_c, "rate_dph": bias_dph(held_c)}
     return {name: np.concatenate([values, after[name]]) for name, values in rows.items()}
 
 
@@ -179,13 +181,13 @@ def test_a_short_exam_states_no_less_than_a_long_one(plain: dict[str, Any], tmp_
     for name, (role, rows) in short.items():
         if role == "exam":
             short[name] = (role, {k: v[: 30 if name != "run-07.csv" else 20] for k, v in rows.items()})
-    some, whole = built(tmp_path, written(tmp_path / "some", short)), plain
-    assert some["evaluate"]["exam"]["samples"] <= 12 and whole["evaluate"]["exam"]["samples"] > 300
-    assert some["budget"]["expanded_dph"] > whole["budget"]["expanded_dph"]
-    known = whole["evaluate"]["uncertainty"]
+    some = built(tmp_path, written(tmp_path / "some", short))
+    assert some["evaluate"]["exam"]["samples"] <= 12 and plain["evaluate"]["exam"]["samples"] > 300
+    assert some["budget"]["expanded_dph"] > plain["budget"]["expanded_dph"]
+    known = plain["evaluate"]["uncertainty"]
     for name, one in (some["evaluate"]["uncertainty"] or {}).items():
         if name in ("rms_dph", "std_dph", "mean_dph", "improvement"):
-            relative = [e["exam"]["after"]["rms_dph"] for e in (some["evaluate"], whole["evaluate"])]
+            relative = [e["exam"]["after"]["rms_dph"] for e in (some["evaluate"], plain["evaluate"])]
             assert one["standard"] / relative[0] > known[name]["standard"] / relative[1], name
 
 

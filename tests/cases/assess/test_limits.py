@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 from typing import Any, Literal
 
@@ -207,13 +208,21 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert not (tmp_path / "three").exists()
 
 
+TARGET = ("--target", "host-gcc-O2")  # without --numeric: the limits file names the arithmetics
+
+
+def built_for(text: str, data: Path, gyrotc: Command) -> tuple[subprocess.CompletedProcess[str], Path]:
+    """Build recordings for the product that a limits file describes; return what the command said, and the result."""
+    product, out = data.parent / "product.toml", data.parent / "out"
+    product.write_text(f"schema = 1\n{text}\n")
+    return gyrotc("build", *TARGET, "--limits", product, data, "--out", out), out
+
+
 def test_a_product_gets_the_arithmetic_and_the_parts_that_it_needs(tmp_path: Path, gyrotc: Command) -> None:
     """What it can do without is not among the files, which are 100 kB at most."""
     recording(tmp_path / "data", "RLG-1")
-    product = tmp_path / "product.toml"
-    product.write_text('schema = 1\n[needs]\narithmetics = ["f32"]\nimage = false\nuncertainty = false\n')
-    out = tmp_path / "out"
-    done = gyrotc("build", "--target", "host-gcc-O2", "--limits", product, tmp_path / "data", "--out", out)
+    needs = '[needs]\narithmetics = ["f32"]\nimage = false\nuncertainty = false'
+    done, out = built_for(needs, tmp_path / "data", gyrotc)
     assert done.returncode == 0, done.stderr
     assert {path.suffix for path in (out / "c").iterdir()} == {".c", ".h", ".bin", ".hex", ".json"}
     assert {path.name for path in (out / "c").glob("*.[ch]")} == {
@@ -226,10 +235,8 @@ def test_a_product_gets_the_arithmetic_and_the_parts_that_it_needs(tmp_path: Pat
 def test_an_arithmetic_that_is_needed_and_refused_misses_its_limit(tmp_path: Path, gyrotc: Command) -> None:
     """The other arithmetic is written all the same, with the reason."""
     recording(tmp_path / "data", "RLG-1")
-    product = tmp_path / "product.toml"
-    product.write_text('schema = 1\nq31_bias_frac_bits = 60\n[needs]\narithmetics = ["q31"]\n')
-    out = tmp_path / "out"
-    done = gyrotc("build", "--target", "host-gcc-O2", "--limits", product, tmp_path / "data", "--out", out)
+    needs = 'q31_bias_frac_bits = 60\n[needs]\narithmetics = ["q31"]'
+    done, out = built_for(needs, tmp_path / "data", gyrotc)
     assert done.returncode == 1 and "limit needs.arithmetics" in done.stderr
     assert (out / "c" / "gtc_f32.c").exists() and not (out / "c" / "gtc_q31.c").exists()
     assert list(json.loads((out / "manifest.json").read_text())["refused"]) == ["q31"]
@@ -241,11 +248,8 @@ def test_the_arithmetic_may_be_refused_for_one_axis_alone(tmp_path: Path, gyrotc
     constants = {"x": 300.0, "y": -20.0, "z": -20.001}
     rates = {f"rate_{axis}_dph": rows["rate_dph"] + constant for axis, constant in constants.items()}
     write_csv(tmp_path / "imu" / "run-01.csv", {name: rows[name] for name in ("time_s", "temperature_c")} | rates)
-    product = tmp_path / "product.toml"
-    product.write_text('schema = 1\nq31_bias_frac_bits = 24\n[needs]\narithmetics = ["q31"]\n')
-    out = tmp_path / "out"
-    host = ("--target", "host-gcc-O2")
-    done = gyrotc("build", *host, "--limits", product, tmp_path / "imu", "--out", out)
+    needs = 'q31_bias_frac_bits = 24\n[needs]\narithmetics = ["q31"]'
+    done, out = built_for(needs, tmp_path / "imu", gyrotc)
     assert done.returncode == 1 and "axis x: limit needs.arithmetics q31 is not met: f32" in done.stderr
     tables = {axis: (out / "c" / f"gtc_imu_{axis}.h").read_text() for axis in "xyz"}
     assert {axis: "gtc_q31_table_t" in text for axis, text in tables.items()} == {"x": False, "y": True, "z": True}
@@ -253,7 +257,7 @@ def test_the_arithmetic_may_be_refused_for_one_axis_alone(tmp_path: Path, gyrotc
     assert [name for name in ("x_f32", "x_q31", "y_f32", "y_q31", "z_q31") if f"&gtc_imu_{name})" in main] == [
         "x_f32", "y_q31", "z_q31",
     ]  # fmt: skip
-    assert gyrotc("verify", out, *host).returncode == 0
+    assert gyrotc("verify", out, *TARGET).returncode == 0
 
 
 _TERM = Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v")

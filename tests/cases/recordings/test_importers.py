@@ -658,21 +658,23 @@ def test_a_column_of_text_that_should_hold_numbers_is_named(tmp_path: Path, run:
     assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1400.0
 
 
+def printed_of(folder: Path, names: str, values: str) -> str:
+    """Return what an import says of a log with more columns; numbers differ from row to row by what replaces `#`."""
+    lines = [f"time_s,temperature_c,rate_dph,{names}"]
+    lines += [f"{k},20.{k},0.0{k},{values.replace('#', str(k))}" for k in range(100, 300)]
+    (folder / "log.csv").write_text("\n".join(lines) + "\n")
+    return run_gyrotc("import", folder / "log.csv", "--serial", "A", "--out", folder / "A").stdout
+
+
 def test_columns_that_an_import_leaves_out_are_named_of_text_as_well(tmp_path: Path) -> None:
-    lines = ["time_s,temperature_c,rate_dph,Status,Volts"]
-    lines += [f"{k},20.{k},0.0{k},OK,5.0{k}" for k in range(100, 300)]
-    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
-    printed = run_gyrotc("import", tmp_path / "log.csv", "--serial", "A", "--out", tmp_path / "A").stdout
+    printed = printed_of(tmp_path, "Status,Volts", "OK,5.0#")
     assert "left out: Volts ([channels] of the map" in printed
     assert "left out: Status (no numbers; --set where" in printed
 
 
 def test_columns_of_one_name_are_named_apart_whatever_the_others_are_called(tmp_path: Path) -> None:
     """The sixth column would be the second "Volts #6"."""
-    lines = ["time_s,temperature_c,rate_dph,Volts #6,Volts,Volts"]
-    lines += [f"{k},20.{k},0.0{k},1.0{k},2.0{k},3.0{k}" for k in range(100, 300)]
-    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
-    printed = run_gyrotc("import", tmp_path / "log.csv", "--serial", "A", "--out", tmp_path / "A").stdout
+    printed = printed_of(tmp_path, "Volts #6,Volts,Volts", "1.0#,2.0#,3.0#")
     assert "left out: Volts #6, Volts, Volts #7 ([channels] of the map" in printed
 
 

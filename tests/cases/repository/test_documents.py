@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -54,15 +55,16 @@ def test_every_option_is_typed_where_a_user_needs_it() -> None:
     pages = [ROOT / "README.md", *(ROOT / "docs" / name for name in re.findall(r"[\w-]+\.md", listed[1]))]
     pages.append(ROOT / "docs" / "tutorial.md")
     commands = get_command(application()).commands  # type: ignore[attr-defined]
-    seen: dict[str, set[str]] = {name: set() for name in commands}
-    for words in (words for page in pages for words in documents.typed(page.read_text("utf-8"))):
-        name = next((word for word in words if word in commands), "") if words[:1] == ["gyrotc"] else ""
-        seen.setdefault(name, set()).update(words)
-    options = {
-        name: [option for option in command.params if option.param_type_name == "option" and option.name != "help"]
+    typed = [words for page in pages for words in documents.typed(page.read_text("utf-8")) if words[:1] == ["gyrotc"]]
+    seen: dict[str, set[str]] = defaultdict(set)
+    for words in typed:
+        seen[next((word for word in words if word in commands), "")].update(words)
+    untyped = {
+        (name, option.opts[0])
         for name, command in commands.items()
+        for option in command.params
+        if option.param_type_name == "option" and option.name != "help" and seen[name].isdisjoint(option.opts)
     }
-    untyped = {(name, o.opts[0]) for name, found in options.items() for o in found if not {*o.opts} & seen[name]}
     assert untyped == set()
 
 

@@ -11,16 +11,17 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
-TEXT = (Path(__file__).resolve().parents[3] / "libc" / "gtc_selftest_f32.h").read_text(encoding="ascii")
+TEXT = (ROOT / "libc" / "gtc_selftest_f32.h").read_text(encoding="ascii")
 LEAST_NORMAL = Fraction(2) ** -126
 ROUND = np.float32(12582912.0)  # F32_ROUND, 1.5 2^23
 
 Float = np.float32
+Pair = tuple[Float, Float]
 ZERO = Float(0)
 
 
@@ -91,7 +92,7 @@ class Arithmetic:
         return np.copysign(Float(float(whole)), Float(-1 if exact < 0 else 1))
 
     def operand(self, x: Float) -> Float:
-        return np.copysign(Float(0), x) if self.flushes_operands and abs(Fraction(float(x))) < LEAST_NORMAL else x
+        return np.copysign(ZERO, x) if self.flushes_operands and abs(Fraction(float(x))) < LEAST_NORMAL else x
 
     def add(self, x: Float, y: Float) -> Float:
         x, y = self.operand(x), self.operand(y)
@@ -111,6 +112,12 @@ class Arithmetic:
             return self.rounded(sign * Fraction(float(x)) * Fraction(float(y)) + Fraction(float(other)))
         return self.add(Float(sign) * self.multiply(x, y), other)
 
+    def sum_of_products(self, first: str, second: str, one: Pair, other: Pair) -> Float:
+        """Return the sum of two products; the one that the name of a fused place begins with is not rounded."""
+        if second in self.fused:
+            one, other, first = other, one, second
+        return self.product_sum(first, *one, self.multiply(*other))
+
     def results(self) -> list[int]:
         """Return the bits of all results in the order of their CRC."""
         found = [
@@ -129,24 +136,17 @@ class Arithmetic:
 
     def _joined(self, a: Float, b: Float, c: Float, d: Float) -> list[Float]:
         eight = Float(8)
-        second = self.multiply(c, d)
-        squares = self.product_sum("a^2 + b^2", a, a, self.multiply(b, b))
-        products = self.product_sum("a b + c d", a, b, second)
-        if "c d + a b" in self.fused:
-            products = self.rounded(Fraction(float(self.multiply(a, b))) + Fraction(float(c)) * Fraction(float(d)))
-        if "b^2 + a^2" in self.fused:
-            squares = self.rounded(Fraction(float(self.multiply(a, a))) + Fraction(float(b)) ** 2)
         shifted = self.product_sum("a b + 8", a, b, eight)
         back = self.add(self.add(a, ROUND), -ROUND)
         return [
             self.product_sum("row: a b + c", a, b, c),
             self.product_sum("row: a b - c", a, b, -c),
             self.product_sum("row: c - a b", a, b, c, -1),
-            products,
-            squares,
+            self.sum_of_products("a b + c d", "c d + a b", (a, b), (c, d)),
+            self.sum_of_products("a^2 + b^2", "b^2 + a^2", (a, a), (b, b)),
             self.multiply(d, self.product_sum("a^2 + c", a, a, c)),
             self.multiply(a, b) if "a b" in self.regrouped else self.add(shifted, -eight),
-            Float(0) if "a - a" in self.regrouped else self.add(a, -back),
+            ZERO if "a - a" in self.regrouped else self.add(a, -back),
         ]
 
     def crc(self) -> int:

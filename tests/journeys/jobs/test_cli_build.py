@@ -242,9 +242,6 @@ def test_a_proven_bound_that_is_exceeded_fails_a_build() -> None:
     assert "q31" in failure and "2e-07" in failure and "1e-07" in failure
 
 
-KILLS = 6
-
-
 def start(folder: Path, out: Path) -> subprocess.Popen[bytes]:
     """The installed command in a process group of its own, so that its compilers end with it."""
     program = Path(sys.executable).with_name("gyrotc")
