@@ -43,7 +43,7 @@ HOST = ("--numeric", "f32", "--target", "host-gcc-O2")
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-# A file that has taken longer, s, begins first: else a worker may be left alone with it at the end.
+# Files that have taken longer than this, s, begin first, so that no worker is left alone with one at the end.
 _LONG_S = 8.0
 _SECONDS_KEPT = "gyrotc/seconds_of_files"
 _seconds: dict[str, float] = {}

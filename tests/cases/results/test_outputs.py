@@ -240,9 +240,7 @@ def test_leftovers_of_dead_jobs_go_and_those_of_others_stay(out: Path) -> None:
 
 
 @pytest.mark.parametrize("renamed", [1, 2])
-def test_a_job_that_is_killed_between_two_renames_is_made_up_for(
-    renamed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_job_that_is_killed_between_two_renames_is_made_up_for(renamed: int, tmp_path: Path) -> None:
     """Where names cannot be exchanged the place is empty for a moment; the next job finds a whole result."""
     out = tmp_path / "out"
     write(out, "one")

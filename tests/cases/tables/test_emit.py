@@ -52,7 +52,7 @@ def test_emitted_files_are_the_golden_ones() -> None:
     assert found == sums
 
 
-def test_emitted_text_names_no_time_path_or_version(tmp_path: Path) -> None:
+def test_emitted_text_names_no_time_path_or_version() -> None:
     from gyrotc import __version__
 
     for name, data in _golden_texts().items():
@@ -131,7 +131,7 @@ def test_main_prints_no_wild_correction_whatever_a_channel_reads(reading: str, t
     assert bias == pytest.approx(expected, abs=2e-6)
 
 
-def test_intel_hex_holds_the_image(tmp_path: Path) -> None:
+def test_intel_hex_holds_the_image() -> None:
     texts = _golden_texts()
     data = bytearray()
     for line in texts["gtc_rlg_0042.hex"].decode().split():

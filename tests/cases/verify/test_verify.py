@@ -516,7 +516,7 @@ def test_a_count_of_random_vectors_that_does_not_fit_is_refused_before_it_is_mad
         pytest.fail(f"{_result(whole, tmp_path, lines)}")
 
 
-def test_one_arithmetic_alone_is_said(whole: Path, run: list[str], tmp_path: Path, gyrotc: Command) -> None:
+def test_one_arithmetic_alone_is_said(run: list[str], tmp_path: Path, gyrotc: Command) -> None:
     copy = emitted(tmp_path / "copy")
     log = tmp_path / "bench.log"
     log.write_text("\n".join(["boot", *run[: _at(run, "begin", "q31") - 1], "done", ""]))

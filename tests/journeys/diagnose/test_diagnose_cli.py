@@ -148,7 +148,7 @@ def test_the_extended_simulation_does_what_the_plain_one_does_not(built: Path) -
 
 
 def test_the_truth_is_not_looked_at(built: Path, tmp_path: Path, gyrotc: Command) -> None:
-    """Without truth.json and truth/ the same result, but for the names of the files."""
+    """Without truth.json and truth/ the result is the same."""
     blind = tmp_path / "blind"
     shutil.copytree(built / "data", blind, ignore=shutil.ignore_patterns("truth*"))
     done = gyrotc("diagnose", blind, "--out", tmp_path / "result")
