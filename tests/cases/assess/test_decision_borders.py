@@ -366,10 +366,12 @@ def test_what_lasts_is_told_from_noise(lasting: float, noise: float) -> None:
 
 
 def test_blocks_that_show_nothing_that_lasts_add_no_degrees_of_freedom() -> None:
-    """Five runs of one mean beside one of three: a single block has products, whose scatter is not known."""
+    """Five runs of one mean beside one of three: the scatter of a single block is not known, that of white noise is."""
     rng = np.random.default_rng(6)
-    one = LastingError.of([averages_of(rng.normal(size=means)) for means in (1, 1, 1, 1, 1, 3)])
+    runs = [rng.normal(size=means) for means in (1, 1, 1, 1, 1, 3)]
+    one = LastingError.of([averages_of(run) for run in runs])
     assert one is not None and one.freedom == 1.0
+    assert one.standard_dph2 == pytest.approx(np.mean(np.concatenate(runs) ** 2) / np.sqrt(3.0)), "of three products"
 
 
 def averages_of(after_dph: Any) -> Averages:
