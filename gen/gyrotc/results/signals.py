@@ -27,10 +27,12 @@ class _State:
 
 def interruption_in(error: BaseException) -> Interrupted | None:
     """Return the signal behind an error: some libraries make an error of their own of whatever ends their import."""
-    behind: BaseException | None = error
-    while behind is not None and not isinstance(behind, Interrupted):
-        behind = behind.__cause__ or behind.__context__
-    return behind
+    behind: list[BaseException] = [error]
+    for one in behind:  # grows by what each was made of; an error may name itself
+        if isinstance(one, Interrupted):
+            return one
+        behind += [e for e in (one.__cause__, one.__context__) if e is not None and e not in behind]
+    return None
 
 
 def raise_on_signals() -> None:

@@ -176,6 +176,15 @@ def test_a_signal_that_a_library_made_an_error_of_is_a_signal(monkeypatch: pytes
         run(["check", "data"])
 
 
+def test_an_error_that_names_itself_as_its_cause_is_an_internal_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(*_arguments: object, **_options: object) -> None:
+        error = ValueError("of itself")
+        raise error from error
+
+    monkeypatch.setattr("gyrotc.cli.main.application", lambda: failing)
+    assert run(["check", "data"]) == 70
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_ctrl_c_is_one_line_and_leaves_nothing(name: str, desk: Path) -> None:
     """At a moment drawn within the first second and a half: imports, work, or its end."""
